@@ -231,7 +231,7 @@ def _regime(
         return regime
     models = [model for view in views for model in design_models(*view, shares)]
     model = next((model for model in models if model.regime == "waves"), models[0])
-    slow = '. Waves may take 100 times as long: optics.psf_model = "rays" is a quick trial'
+    slow = '. Waves may take 50 times as long: optics.psf_model = "rays" is a quick trial'
     note(f"PSF by {model.reason}{slow if model.regime == 'waves' else ''}")
     return model.regime
 

@@ -67,7 +67,7 @@ class OpticsRecipe:
         azimuths_deg: Directions of the fields from +y towards +x, traced through the whole pupil,
             as a lens that is not round needs. Empty for +y alone.
         psf_model: Model of the PSF; empty for waves where the blur of the lens at the start is
-            below 7 Airy radii, else rays. A step by waves may take 100 times as long: begin with
+            below 7 Airy radii, else rays. A step by waves may take 50 times as long: begin with
             `rays`. `azimuths_deg` takes no waves.
     """
 

@@ -119,6 +119,7 @@ class DesignRun:
         if self.loop.step == 0:
             first = self.loop.judge()
             self._refuse_lost(first)
+            first = replace(first, seconds=self.files.stop())
             self._record(first)
             yield first
         for moment in self.loop.run(last_step, on_step):
