@@ -122,8 +122,10 @@ def _take_steps(run: "DesignRun", pictures: int) -> None:
     plan, total, drawn_step = run.recipe, run.recipe.schedule.steps, run.loop.step
     with working(f"designing {plan.name}", total, unit="steps") as task:
         task.begin(run.loop.step)
+        is_saved = run.files.resumes
         try:
             for moment in run.go(on_step=task.count):
+                is_saved = True
                 say(_line(moment, is_psnr=plan.loss.is_psnr) + left_text(task), err=True)
                 if moment.step == 0:
                     _note_limits(run, moment)
@@ -133,7 +135,7 @@ def _take_steps(run: "DesignRun", pictures: int) -> None:
                     _draw(run, moment)
                     drawn_step = moment.step
         except KeyboardInterrupt:
-            if run.leads and run.files.checkpoint.exists():
+            if run.leads and is_saved:
                 say(
                     f"{run.files.checkpoint} is kept: the same command with --resume, without "
                     "--overwrite, continues it",
