@@ -148,6 +148,17 @@ def typed(where: str, value: Any, kind: Any) -> Any:
     return value
 
 
+def check_least(table: Any, least: float, *names: str) -> None:
+    """Refuse attributes of a dataclass that are below the least value.
+
+    Raises:
+        ContractError: Naming the first one.
+    """
+    for name in names:
+        if not (value := getattr(table, name)) >= least:
+            raise ContractError(f"{name} must be >= {least:g}; got {value}")
+
+
 def table_digest(table: Mapping[str, Any]) -> str:
     """Return the sha256 of plain values, whatever the order of their keys."""
     return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()

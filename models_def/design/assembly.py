@@ -27,7 +27,7 @@ from camkit.models_def.design.starts import Starts, best_judged, found_starts
 from camkit.models_def.design.states_module import StatesModule
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.networks.catalog import build_network, check_patch
-from camkit.models_def.optics.analysis.psf_model import checked_regime
+from camkit.models_def.optics.analysis.psf_model import PsfRegime, checked_regime
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.lens_file.states import plain_lens
 from camkit.models_def.optics.optics_file import ALL, state_names
@@ -42,6 +42,7 @@ from camkit.models_def.optics.trace import surface_tensors
 from camkit.models_def.training.first_weights import read_first_weights, take_first_weights
 from camkit.models_def.training.kind import read_recipe
 from camkit.models_def.training.pictures import SceneSource, open_scenes
+from camkit.progress import note
 from camkit.units import to_radians
 
 
@@ -59,6 +60,7 @@ def problem_of(recipe: DesignRecipe, lens: Lens) -> Problem:
             f"optics.solved_surface must be 0..{count - 1} (-1 is the last); got {solved}"
         )
     last = solved % count
+    _refuse_steep_bounds(recipe, lens)
     free = FreeLens(
         lens=lens,
         variables=recipe.variables,
@@ -67,6 +69,50 @@ def problem_of(recipe: DesignRecipe, lens: Lens) -> Problem:
         rides=optics.rides,
     )
     return _problem_at(recipe, free, field_slopes(optics))
+
+
+def _refuse_steep_bounds(recipe: DesignRecipe, lens: Lens) -> None:
+    """Refuse curvatures with which a surface ends within its rim, whatever its conic becomes."""
+    conics = {v.surface: v.low for v in recipe.variables if v.kind == "conic"}
+    for v in recipe.variables:
+        if v.kind != "curvature" or not 0 <= v.surface < len(lens.surfaces):
+            continue
+        surface = lens.surfaces[v.surface]
+        least = 0.0 if v.low <= 0 <= v.high else min(abs(v.low), abs(v.high))
+        shape = max(0.0, 1 + min(surface.conic, conics.get(v.surface, surface.conic)))
+        rim_mm = surface.semi_diameter_mm
+        if math.isfinite(rim_mm) and least * rim_mm * math.sqrt(shape) >= 1:
+            raise ContractError(
+                f"curvature of surface {v.surface}: {v.low:g} .. {v.high:g} 1/mm cannot reach its "
+                f"rim, {rim_mm:g} mm from the axis. A curvature is 1 / radius, in 1/mm: give "
+                "vary.low and vary.high so"
+            )
+
+
+def refuse_small_image(recipe: DesignRecipe, problem: Problem) -> None:
+    """Refuse fields whose whole image is smaller than one patch with its PSF.
+
+    Raises:
+        ContractError: Naming the keys that say how large the image is.
+    """
+    optics, pixels = recipe.optics, recipe.pixels
+    free = problem.free
+    reference_um = torch.tensor([free.lens.reference_wavelength_um], dtype=torch.float64)
+    reference = free.tensors(free.scaled()[None], reference_um)
+    scale_mm = abs(float(image_scale_mm(reference, problem.depths_mm[0])))
+    height_mm = scale_mm * float(problem.slopes.max())
+    width_px, side_px = (
+        2000 * height_mm / pixels.pitch_um,
+        recipe.schedule.patch_px + max(0, pixels.kernel_px - 1),
+    )
+    if width_px < side_px:
+        efl_text = f" and efl_mm = {optics.efl_mm:g}" if optics.efl_mm else ""
+        raise ContractError(
+            f"optics.half_field_deg = {optics.half_field_deg:g} degrees{efl_text} make an image "
+            f"{2 * height_mm:.3g} mm wide, {width_px:.3g} px of pixels.pitch_um = "
+            f"{pixels.pitch_um:g} um; a patch with its PSF takes {side_px} px. Check the units of "
+            "these keys"
+        )
 
 
 def joint_problem_of(recipe: DesignRecipe, lens: Lens) -> JointProblem:
@@ -165,21 +211,29 @@ def pixels_of(recipe: DesignRecipe, *views: tuple[Problem, Tensor]) -> Pixels:
         color_weights=weights / weights.sum(1, keepdim=True),
         window_follows=recipe.camera is not None,
     )
-    regime = checked_regime(recipe.optics.psf_model, "optics.psf_model")
-    if any(problem.whole_pupil for problem, _ in views):
-        regime = "rays"
-    if regime is None:
-        models = [
-            model
-            for problem, begin in views
-            for model in design_models(problem, begin, pixels.color_weights)
-        ]
-        regime = "waves" if any(model.regime == "waves" for model in models) else "rays"
-    pixels = replace(pixels, regime=regime)
+    pixels = replace(pixels, regime=_regime(recipe, views, pixels.color_weights))
     if recipe.pixels.kernel_px:
         return pixels
     windows = [fitting_window_px(problem, begin, pixels) for problem, begin in views]
     return replace(pixels, kernel_px=max(windows))
+
+
+def _regime(
+    recipe: DesignRecipe, views: Sequence[tuple[Problem, Tensor]], shares: Tensor
+) -> PsfRegime:
+    """Return the PSF model of a recipe, and note the reason."""
+    regime = checked_regime(recipe.optics.psf_model, "optics.psf_model")
+    if any(problem.whole_pupil for problem, _ in views):
+        note("PSF by rays: azimuths_deg takes no waves")
+        return "rays"
+    if regime is not None:
+        note(f"PSF by {regime}: optics.psf_model of the recipe")
+        return regime
+    models = [model for view in views for model in design_models(*view, shares)]
+    model = next((model for model in models if model.regime == "waves"), models[0])
+    slow = '. Waves may take 50 times as long: optics.psf_model = "rays" is a quick trial'
+    note(f"PSF by {model.reason}{slow if model.regime == 'waves' else ''}")
+    return model.regime
 
 
 def recorder_of(recipe: DesignRecipe) -> Recorder:
@@ -269,6 +323,7 @@ def parts_of(
         states = find_lens(recipe.prescription, folder, with_states=True)
         return parts_at(_states_module(recipe, states), network_of(recipe))
     problem = problem_of(recipe, find_lens(recipe.prescription, folder))
+    refuse_small_image(recipe, problem)
     plan = recipe.starts if recipe.schedule.lens_rate else Starts()
     shipped = [library_start(problem, start)] if start else []
     starts = shipped or found_starts(problem, plan)

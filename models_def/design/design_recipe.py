@@ -1,16 +1,16 @@
 """A joint design as TOML: which lens, what of it is free, what it looks at, what recovers it."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Final, Literal, TypeVar, get_args
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, UnsupportedError
+from camkit.models_def.design.design_schedule import DesignSchedule
 from camkit.models_def.design.expected import Descent
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.lens_module import MoveUnits
-from camkit.models_def.design.loop import DesignSchedule
 from camkit.models_def.design.loss import DesignLoss
 from camkit.models_def.design.shipped_camera import CameraChoice
 from camkit.models_def.design.starts import Starts
@@ -21,7 +21,14 @@ from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.variables import Variable
 from camkit.models_def.optics.shape.phase import Phase, parse_monomials
 from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors
-from camkit.models_def.toml_table import check_keys, faults_of, section, table_digest, typed
+from camkit.models_def.toml_table import (
+    check_keys,
+    check_least,
+    faults_of,
+    section,
+    table_digest,
+    typed,
+)
 from camkit.models_def.training.recipe import SceneRecipe
 from camkit.side_file import read_side_toml
 
@@ -49,7 +56,7 @@ class OpticsRecipe:
         solved_surface: Surface whose curvature keeps `efl_mm`, from 0; -1 is the last one. Its
             curvature is not free.
         rides: The sensor follows the paraxial image. If false, free the last gap.
-        pupil_rays: Number of rays in half the pupil.
+        pupil_rays: Number of rays in half the pupil; at least 1.
         whiten: One unit of every move changes the RMS spot by one pixel, so that one
             `lens_rate` serves all numbers.
         units: Unit of a move where `whiten` is false. `range`: the whole range of a number.
@@ -60,7 +67,8 @@ class OpticsRecipe:
         azimuths_deg: Directions of the fields from +y towards +x, traced through the whole pupil,
             as a lens that is not round needs. Empty for +y alone.
         psf_model: Model of the PSF; empty for waves where the blur of the lens at the start is
-            below 7 Airy radii, else rays. `azimuths_deg` takes no waves.
+            below 7 Airy radii, else rays. A step by waves may take 50 times as long: begin with
+            `rays`. `azimuths_deg` takes no waves.
     """
 
     half_field_deg: float
@@ -80,10 +88,12 @@ class OpticsRecipe:
     psf_model: str = ""
 
     def __post_init__(self) -> None:
-        if not 0 < self.half_field_deg < 80 or self.fields < 2 or self.pupil_rays < 1:
+        if not 0 < self.half_field_deg < 80:
             raise ContractError(
-                "optics needs half_field_deg in 0..80, fields >= 2 and pupil_rays >= 1"
+                f"half_field_deg must be > 0 and < 80 degrees; got {self.half_field_deg}"
             )
+        check_least(self, 2, "fields")
+        check_least(self, 1, "pupil_rays")
         if self.spacing not in get_args(Spacing):
             raise ContractError(
                 f"spacing must be one of {', '.join(get_args(Spacing))}; got {self.spacing!r}"
@@ -168,6 +178,8 @@ class PixelRecipe:
     cfa: str = ""
 
     def __post_init__(self) -> None:
+        if not self.pitch_um > 0:
+            raise ContractError(f"pitch_um must be > 0; got {self.pitch_um}")
         rows = {len(row) for row in self.color_weights}
         if len(self.color_weights) != 3 or rows != {len(self.wavelengths_um)}:
             raise ContractError(
@@ -285,16 +297,16 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
         prescription=typed("prescription", table["prescription"], str),
         variables=tuple(v.variable for v in variables if not v.state),
         state_variables=tuple(v for v in variables if v.state),
-        phases=tuple(section(f"phase[{i}]", PhaseRecipe, p) for i, p in enumerate(phases)),
-        optics=section("optics", OpticsRecipe, table["optics"]),
-        limits=section("limits", Limits, table.get("limits", {})),
-        pixels=section("pixels", PixelRecipe, table["pixels"]),
-        front=section("front", Front, table.get("front", {})),
-        network=section("network", NetworkChoice, table.get("network", {})),
-        loss=section("loss", DesignLoss, table.get("loss", {})),
-        schedule=section("schedule", DesignSchedule, table.get("schedule", {})),
-        data=section("data", SceneRecipe, table.get("data", {})),
-        starts=section("starts", Starts, table.get("starts", {})),
+        phases=tuple(_table(f"phase[{i}]", PhaseRecipe, p) for i, p in enumerate(phases)),
+        optics=_table("optics", OpticsRecipe, table["optics"]),
+        limits=_table("limits", Limits, table.get("limits", {})),
+        pixels=_table("pixels", PixelRecipe, table["pixels"]),
+        front=_table("front", Front, table.get("front", {})),
+        network=_table("network", NetworkChoice, table.get("network", {})),
+        loss=_table("loss", DesignLoss, table.get("loss", {})),
+        schedule=_table("schedule", DesignSchedule, table.get("schedule", {})),
+        data=_table("data", SceneRecipe, table.get("data", {})),
+        starts=_table("starts", Starts, table.get("starts", {})),
         fabrication=_optional("fabrication", FabricationErrors, table),
         camera=_optional("camera", CameraChoice, table),
         descent=_optional("descent", Descent, table),
@@ -313,11 +325,23 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
 
 def _variable(where: str, table: Any) -> JointVariable:
     """Read a free number, and the configuration that it is of, if any."""
+    if isinstance(table, Mapping):
+        check_keys(where, table, {STATE_KEY, *(one.name for one in fields(Variable))})
     if not isinstance(table, Mapping) or STATE_KEY not in table:
-        return JointVariable(variable=section(where, Variable, table))
+        return JointVariable(variable=_table(where, Variable, table))
     state = typed(f"{where}.{STATE_KEY}", table[STATE_KEY], str)
     rest = {key: value for key, value in table.items() if key != STATE_KEY}
-    return JointVariable(variable=section(where, Variable, rest), state=state)
+    return JointVariable(variable=_table(where, Variable, rest), state=state)
+
+
+def _table(where: str, kind: type[T], table: Any) -> T:
+    """Read a table; a message that begins with one of its keys names the table too."""
+    try:
+        return section(where, kind, table)
+    except ContractError as error:
+        if str(error).split(" ")[0] in {one.name for one in fields(kind)}:  # type: ignore[arg-type]
+            raise ContractError(f"{where}.{error}") from error
+        raise
 
 
 def _check_states(recipe: DesignRecipe) -> None:
@@ -335,7 +359,7 @@ def _check_states(recipe: DesignRecipe) -> None:
 
 
 def _optional(name: str, kind: type[T], table: Mapping[str, Any]) -> T | None:
-    return section(name, kind, table[name]) if name in table else None
+    return _table(name, kind, table[name]) if name in table else None
 
 
 def with_choices(

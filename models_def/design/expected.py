@@ -24,6 +24,7 @@ from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.design.shipped_camera import Camera
 from camkit.models_def.sensors.together import CORNER_FREQUENCY, frequencies_squared
 from camkit.models_def.sensors.wiener import to_otf
+from camkit.models_def.toml_table import check_least
 
 GRID_PX: Final = 96
 """Side of the grid of frequencies; a kernel that is wider wraps, which keeps its transfer there."""
@@ -65,12 +66,12 @@ class Descent:
     penalty_weight: float = 50.0
 
     def __post_init__(self) -> None:
-        if min(self.rounds, self.evaluations, self.starts, self.copies) < 1 or not self.iso:
-            raise ContractError(f"counts of a descent must be >= 1; got {self}")
-        if not (min(self.iso) > 0 and self.level > 0 and min(self.spread, self.evenness) >= 0):
-            raise ContractError(
-                f"descent.iso and level must be > 0, spread and evenness >= 0; got {self}"
-            )
+        check_least(self, 1, "rounds", "evaluations", "starts", "copies")
+        check_least(self, 0, "spread", "evenness")
+        if not min(self.iso, default=0.0) > 0:
+            raise ContractError(f"iso must be numbers > 0; got {list(self.iso)}")
+        if not self.level > 0:
+            raise ContractError(f"level must be > 0; got {self.level}")
 
 
 class ExpectedError:

@@ -11,7 +11,7 @@ draws its own patches, gradients are averaged.
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -19,7 +19,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from camkit.errors import ContractError
+from camkit.models_def.design.design_schedule import DesignSchedule
 from camkit.models_def.design.fabrication import draw_copy
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.lens import DesignLens
@@ -38,50 +38,7 @@ SPREAD_SEED: Final = 980_000
 _CLIP: Final = 1.0
 
 State = dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignSchedule:
-    """The schedule of a design.
-
-    Attributes:
-        steps: Number of steps.
-        batch: Patches of a step.
-        patch_px: Side of a patch after blur and margins; a multiple of the network's stride.
-        lens_rate: Learning rate of the lens; 0 trains the network alone.
-        network_rate: Learning rate of the network.
-        epoch_steps: Steps after which both rates are multiplied by `decay`.
-        decay: Factor of both rates after every `epoch_steps`; more than 0, at most 1.
-        hold_steps: First steps in which the lens stays, until the network follows.
-        freeze_share: Last share of the steps in which the lens stays, 0 to 1.
-        penalty_weight: Weight of `[limits]` in the loss.
-        valid_steps: Steps between validations.
-        valid_patches: Fixed patches of a validation.
-        seed: Random seed of weights and samples.
-    """
-
-    steps: int = 2000
-    batch: int = 8
-    patch_px: int = 128
-    lens_rate: float = 0.02
-    network_rate: float = 8e-4
-    epoch_steps: int = 200
-    decay: float = 0.8
-    hold_steps: int = 100
-    freeze_share: float = 0.25
-    penalty_weight: float = 10.0
-    valid_steps: int = 100
-    valid_patches: int = 24
-    seed: int = 1
-
-    def __post_init__(self) -> None:
-        counts = (self.steps, self.batch, self.patch_px, self.epoch_steps, self.valid_steps)
-        if min(*counts, self.valid_patches) < 1:
-            raise ContractError(f"counts of a design schedule must be >= 1; got {self}")
-        if not (0 <= self.freeze_share <= 1 and 0 < self.decay <= 1):
-            raise ContractError(f"freeze_share and decay must lie in 0..1; got {self}")
-        if min(self.lens_rate, self.network_rate) < 0:
-            raise ContractError(f"learning rates must be >= 0; got {self}")
+Watch = Callable[[int], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,6 +97,9 @@ class Progress:
         loss: Of the last step.
         valid_db: Mean PSNR of sRGB values over fixed patches.
         best_db: That of the best lens so far.
+        merit: What the best lens has the most of, see `DesignLoop.judge`.
+        best_merit: That of the best lens so far.
+        best_step: Steps that the best lens had done.
         lost_light: Share outside the window of a kernel, at the worst field, depth and colour.
     """
 
@@ -148,6 +108,9 @@ class Progress:
     loss: float
     valid_db: float
     best_db: float
+    merit: float
+    best_merit: float
+    best_step: int
     lost_light: float
 
 
@@ -159,6 +122,7 @@ class DesignLoop:
         self.step = 0
         self.best_db = -math.inf
         self.best_merit = -math.inf
+        self.best_step = 0
         self.best: State = {}
         self._spread: Tensor | None = None
         groups = [{"params": [parts.lens.moves], "lr": schedule.lens_rate}]
@@ -168,18 +132,25 @@ class DesignLoop:
         self._optimizer = torch.optim.Adam(groups)
         self._valid = [self._draw(VALID_SEED + i, 1) for i in range(schedule.valid_patches)]
 
-    def run(self, last_step: int | None = None) -> Iterator[Progress]:
-        """Run up to a step (the last by default), yielding every validated moment."""
+    def run(self, last_step: int | None = None, on_step: Watch | None = None) -> Iterator[Progress]:
+        """Run up to a step (the last by default), yielding every validated moment.
+
+        Args:
+            last_step: To run up to.
+            on_step: Is called with the number of finished steps after each one.
+        """
         schedule, begin = self.schedule, time.monotonic()
         end = schedule.steps if last_step is None else min(last_step, schedule.steps)
         while self.step < end:
             loss = self._one_step()
+            if on_step is not None:
+                on_step(self.step)
             if self.step % schedule.valid_steps == 0 or self.step == end:
                 yield self.judge(loss, time.monotonic() - begin)
 
     def _one_step(self) -> float:
         schedule, parts = self.schedule, self.parts
-        moving = self._lens_moves()
+        moving = schedule.moves_lens(self.step, has_network=parts.network is not None)
         decay = schedule.decay ** (self.step // schedule.epoch_steps)
         for group, rate in zip(self._optimizer.param_groups, self._rates, strict=True):
             group["lr"] = rate * decay
@@ -206,11 +177,6 @@ class DesignLoop:
         self._optimizer.step()
         self.step += 1
         return float(loss.detach())
-
-    def _lens_moves(self) -> bool:
-        schedule = self.schedule
-        last = schedule.steps - round(schedule.freeze_share * schedule.steps)
-        return schedule.lens_rate > 0 and schedule.hold_steps <= self.step < last
 
     def _kernels(self, *, moving: bool) -> tuple[Tensor, Tensor]:
         with torch.set_grad_enabled(moving):
@@ -331,12 +297,16 @@ class DesignLoop:
         merit -= self.schedule.penalty_weight * float(penalty)
         if merit > self.best_merit:
             self.best_db, self.best_merit, self.best = valid_db, merit, self._weights()
+            self.best_step = self.step
         return Progress(
             step=self.step,
             seconds=seconds,
             loss=loss,
             valid_db=valid_db,
             best_db=self.best_db,
+            merit=merit,
+            best_merit=self.best_merit,
+            best_step=self.best_step,
             lost_light=1 - float(knowledge.kernels.sum((-2, -1)).amin()),
         )
 
@@ -421,6 +391,7 @@ class DesignLoop:
             "step": self.step,
             "best_db": self.best_db,
             "best_merit": self.best_merit,
+            "best_step": self.best_step,
             "best": self.best,
             "weights": self._weights(),
             "optimizer": self._optimizer.state_dict(),
@@ -430,6 +401,7 @@ class DesignLoop:
         """Restore a saved state."""
         self.step, self.best = state["step"], state["best"]
         self.best_db, self.best_merit = state["best_db"], state["best_merit"]
+        self.best_step = state.get("best_step", 0)
         self._spread = state.get("spread")
         self._set(state["weights"])
         self._optimizer.load_state_dict(state["optimizer"])

@@ -10,10 +10,11 @@ from typing import Any, Final
 import torch
 from torch import Tensor, nn
 
+from camkit.errors import ContractError
 from camkit.models_def.design.assembly import parts_of
 from camkit.models_def.design.design_recipe import DesignRecipe, recipe_digest
 from camkit.models_def.design.lens import DesignLens
-from camkit.models_def.design.loop import DesignLoop, DesignParts, Progress
+from camkit.models_def.design.loop import DesignLoop, DesignParts, Progress, Watch
 from camkit.models_def.design.run_files import RunFiles, RunOptions
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.optics.lens_file.lens_file import write_lens
@@ -23,6 +24,8 @@ from camkit.models_def.optics.search.problem import valid_share
 from camkit.models_def.training.log import read_log
 
 FORMAT: Final = 2
+_LEAST_RAYS: Final = 0.5
+_MOST_LOST: Final = 0.99
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,15 +105,49 @@ class DesignRun:
         """Return whether this process writes the files."""
         return not torch.distributed.is_initialized() or torch.distributed.get_rank() == 0
 
-    def go(self, last_step: int | None = None) -> Iterator[Progress]:
-        """Run, yielding every validated moment after it is on disk."""
+    def go(self, last_step: int | None = None, on_step: Watch | None = None) -> Iterator[Progress]:
+        """Run, yielding every validated moment, the beginning included, after it is on disk.
+
+        Args:
+            last_step: To run up to; the last by default.
+            on_step: Is called with the number of finished steps after each one.
+
+        Raises:
+            ContractError: If most rays of the lens at the start are lost, or all light of a field.
+        """
         self.files.start()
         if self.loop.step == 0:
-            self._record(self.loop.judge())
-        for moment in self.loop.run(last_step):
+            first = self.loop.judge()
+            self._refuse_lost(first)
+            first = replace(first, seconds=self.files.stop())
+            self._record(first)
+            yield first
+        for moment in self.loop.run(last_step, on_step):
             timed = replace(moment, seconds=self.files.stop())
             self._record(timed)
             yield timed
+
+    def _refuse_lost(self, first: Progress) -> None:
+        """Refuse a start whose gradients say nothing: a unit of the recipe is likely wrong."""
+        lens, optics = self.loop.parts.lens, self.recipe.optics
+        ray_share = _valid_rays(lens)
+        if ray_share < _LEAST_RAYS:
+            raise ContractError(
+                f"{ray_share:.0%} of the rays reach the sensor at the start. Check the bounds of "
+                f"[[vary]] (a curvature is 1 / radius, in 1/mm), optics.half_field_deg = "
+                f"{optics.half_field_deg:g} degrees, efl_mm = {optics.efl_mm:g} and f_number = "
+                f"{optics.f_number:g}, or begin at another lens"
+            )
+        if first.lost_light > _MOST_LOST:
+            pixels = lens.pixels
+            width_um = pixels.kernel_px * pixels.pitch_um
+            raise ContractError(
+                f"{first.lost_light:.0%} of the light of the worst field falls beyond the window "
+                f"of the PSF at the start: {pixels.kernel_px} px (pixels.kernel_px) of "
+                f"{pixels.pitch_um:g} um (pixels.pitch_um) are {width_um:.3g} um. Check pitch_um, "
+                f"the bounds of [[vary]] and optics.half_field_deg = {optics.half_field_deg:g} "
+                "degrees, begin at a sharper lens, or take a larger kernel_px"
+            )
 
     def _record(self, moment: Progress) -> None:
         if not self.leads:
@@ -121,6 +158,7 @@ class DesignRun:
             "loss": moment.loss if math.isfinite(moment.loss) else None,
             "valid_db": moment.valid_db,
             "best_db": moment.best_db,
+            "merit": moment.merit,
             "lost_light": moment.lost_light,
             "valid_rays": _valid_rays(lens),
         }
@@ -129,6 +167,7 @@ class DesignRun:
 
     def finish(self) -> dict[str, Any]:
         """Restore the best lens, write it, and return a report on the run."""
+        begin = read_log(self.files.log)[0]
         self.loop.take_best()
         lens = self.loop.parts.lens
         best_lens = lens.finished()
@@ -139,8 +178,12 @@ class DesignRun:
             "start": self.loop.parts.start or self.recipe.prescription,
             "steps": self.loop.step,
             "psf_model": "waves" if bool(lens.state_dict()["sharp"].any()) else "rays",
-            "begin_db": read_log(self.files.log)[0]["valid_db"],
+            "begin_db": begin["valid_db"],
             "best_db": self.loop.best_db,
+            "best_step": self.loop.best_step,
+            "begin_merit": begin.get("merit"),
+            "best_merit": self.loop.best_merit,
+            "is_psnr": self.recipe.loss.is_psnr,
             "seconds": round(self.files.spent_s, 1),
             "cpu_s": round(self.files.spent_cpu_s, 1),
             "lens": str(self.lens_file),

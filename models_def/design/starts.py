@@ -24,6 +24,7 @@ from camkit.models_def.optics.search.improvement import Improvement, improve
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.spot_residuals import MERITS, Merit
 from camkit.models_def.optics.search.variables import FreeLens
+from camkit.models_def.toml_table import check_least
 
 T = TypeVar("T")
 
@@ -70,15 +71,12 @@ class Starts:
     elements: int = 0
 
     def __post_init__(self) -> None:
-        counts = (self.count, self.scout_steps, self.dls_steps, self.judged)
-        least = min(*counts, self.core_um, self.depth_mm)
-        if self.library_lenses < 1 or self.elements < 0:
-            raise ContractError(f"starts needs library_lenses >= 1 and elements >= 0; got {self}")
-        if least < 0 or not (0 <= self.spread <= 1 and 0 <= self.anywhere <= 1):
-            raise ContractError(
-                "starts needs counts >= 0, core_um and depth_mm >= 0, spread and anywhere in 0..1; "
-                f"got {self}"
-            )
+        check_least(self, 0, "count", "scout_steps", "dls_steps", "judged", "elements")
+        check_least(self, 0, "core_um", "depth_mm", "spread", "anywhere")
+        check_least(self, 1, "library_lenses")
+        for name in ("spread", "anywhere"):
+            if getattr(self, name) > 1:
+                raise ContractError(f"{name} must lie in 0..1; got {getattr(self, name)}")
         if self.merit not in MERITS:
             raise ContractError(f"starts.merit is one of {', '.join(MERITS)}; got {self.merit!r}")
         if self.judged and not 2 <= self.judged <= self.ends:

@@ -51,7 +51,7 @@ vary = [
 ]
 
 [optics]
-half_field_deg = 20.0
+half_field_deg = 12.0
 efl_mm = 50.0
 
 [pixels]

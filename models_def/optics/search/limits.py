@@ -40,7 +40,10 @@ class Limits:
 
     def __post_init__(self) -> None:
         if not (self.distortion > 0 and self.max_curvature_per_mm > 0):
-            raise ContractError(f"distortion and curvature limits must be > 0; got {self}")
+            raise ContractError(
+                "distortion and max_curvature_per_mm must be > 0; got "
+                f"{self.distortion:g} and {self.max_curvature_per_mm:g}"
+            )
 
 
 def limit_residuals(
@@ -50,8 +53,10 @@ def limit_residuals(
     *,
     solved: int | None,
     glass: tuple[bool, ...],
-) -> Tensor:
-    """Return residuals (start, residual). Thickness at the centre is a matter of bounds.
+) -> dict[str, Tensor]:
+    """Return residuals (start, residual) by the keys of `Limits` that they hold.
+
+    Thickness at the centre is a matter of bounds.
 
     Args:
         limits: The limits.
@@ -70,12 +75,12 @@ def limit_residuals(
     thin = torch.relu(torch.tensor(least, dtype=gaps.dtype)[:, None] - edges)
     steep = torch.relu(steepness(curvature, rho) - limits.max_steepness)
     short = torch.relu(limits.min_bfl_mm - gaps[-1])[None]
-    rows = [thin, steep, short]
+    rows = {"min_edge_mm or min_air_mm": thin, "max_steepness": steep, "min_bfl_mm": short}
     if solved is not None:
-        rows.append(
+        rows["max_curvature_per_mm"] = (
             torch.relu(torch.abs(curvature[solved]) - limits.max_curvature_per_mm)[None] * 10
         )
-    return torch.cat([row.T for row in rows], dim=1) * _PENALTY_PER_MM
+    return {key: row.T * _PENALTY_PER_MM for key, row in rows.items()}
 
 
 def steepness(curvature: Tensor, rho: list[Tensor]) -> Tensor:

@@ -189,27 +189,40 @@ def residuals(problem: Problem, scaled: Tensor) -> Tensor:
 
 def limits_of(problem: Problem, traced: Traced, distance_mm: float) -> Tensor:
     """Return residuals (start, residual) of what the lenses must not be."""
+    return torch.cat([*_limit_parts(problem, traced, distance_mm).values()], dim=1)
+
+
+def broken_limits(problem: Problem, scaled: Tensor) -> dict[str, float]:
+    """Return what a lens (variable,) pays for each limit that it breaks, as a sum of squares."""
+    distance_mm = problem.limited_mm
+    with torch.no_grad():
+        traced = trace_batch(problem, scaled[None], distance_mm)
+        parts = _limit_parts(problem, traced, distance_mm)
+    costs = {key: float(part.square().sum()) for key, part in parts.items()}
+    return {key: cost for key, cost in costs.items() if cost > 0}
+
+
+def _limit_parts(problem: Problem, traced: Traced, distance_mm: float) -> dict[str, Tensor]:
+    """Return the residuals (start, residual) of the limits by key; rays have none."""
     free, limits = problem.free, problem.limits
-    parts = [
-        limit_residuals(
-            limits,
-            traced.tensors,
-            traced.surface_rays,
-            solved=free.solved,
-            glass=tuple(s.glass != "air" for s in free.lens.surfaces),
-        ),
-        ray_residuals(
-            traced.tensors,
-            leading(traced.launched),
-            [leading(rays) for rays in traced.surface_rays],
-        ),
-    ]
+    parts = limit_residuals(
+        limits,
+        traced.tensors,
+        traced.surface_rays,
+        solved=free.solved,
+        glass=tuple(s.glass != "air" for s in free.lens.surfaces),
+    )
+    parts["rays that are lost, or nearly"] = ray_residuals(
+        traced.tensors,
+        leading(traced.launched),
+        [leading(rays) for rays in traced.surface_rays],
+    )
     if math.isfinite(limits.distortion) and len(problem.slopes) > 1:
         middle = len(problem.wavelengths_um) // 2
         chief = _radial(problem, traced.landings)[:, 1:, middle]
         ideal = problem.slopes[1:] * image_scale_mm(traced.reference, distance_mm)
-        parts.append(distortion_residuals(limits, chief, ideal))
-    return torch.cat(parts, dim=1)
+        parts["distortion"] = distortion_residuals(limits, chief, ideal)
+    return parts
 
 
 def _radial(problem: Problem, landings: Rays) -> Tensor:

@@ -72,7 +72,9 @@ class Variable:
         if self.kind not in PARAMETERS:
             raise ContractError(f"a variable is one of {', '.join(PARAMETERS)}; got {self.kind!r}")
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low <= self.high):
-            raise ContractError(f"a variable needs bounds low <= high; got {self}")
+            raise ContractError(
+                f"low must be <= high, both finite; got low = {self.low:g}, high = {self.high:g}"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,12 +100,19 @@ class FreeLens:
         count, places = len(self.lens.surfaces), set()
         for variable in self.variables:
             place = (variable.kind, variable.surface, variable.term)
-            if not 0 <= variable.surface < count or place in places:
-                raise ContractError(f"a variable needs a surface of its own; got {variable}")
+            what = f"{variable.kind} of surface {variable.surface}"
+            if not 0 <= variable.surface < count:
+                raise ContractError(
+                    f"{what}: the lens has {count} surfaces, 0..{count - 1}; a variable needs one"
+                )
+            if place in places:
+                raise ContractError(f"{what}, term {variable.term}, is listed twice as free")
             places.add(place)
             self._check_term(variable)
             if variable.kind == "curvature" and variable.surface == self.solved:
-                raise ContractError(f"the curvature of surface {self.solved} is solved: not free")
+                raise ContractError(
+                    f"{what} is solved for the focal length (solved_surface): it is not free"
+                )
             last = variable.kind == "thickness" and variable.surface == count - 1
             if last and self.rides:
                 raise ContractError("the sensor rides on the image: free its defocus instead")
@@ -121,7 +130,10 @@ class FreeLens:
             "phase": variable.term < len(phase_terms),
         }
         if not fits.get(variable.kind, True):
-            raise ContractError(f"surface {variable.surface} has no such term; got {variable}")
+            raise ContractError(
+                f"surface {variable.surface} has no such term; got {variable.kind}, term "
+                f"{variable.term}"
+            )
 
     @property
     def is_round(self) -> bool:

@@ -107,7 +107,20 @@ def change(key: str, **entries: Any) -> Callable[[dict[str, Any]], None]:
         (change("front", kind="magic"), "one of none, wiener"),
         (change("loss", kind="l7"), "one of"),
         (change("network", name="resnet"), "network must be one of"),
-        (change("schedule", steps=0), "must be >= 1"),
+        (change("schedule", steps=0), r"schedule\.steps must be >= 1; got 0"),
+        (change("schedule", hold_steps=-1), r"schedule\.hold_steps must be >= 0; got -1"),
+        (change("optics", fields=1), r"optics\.fields must be >= 2; got 1"),
+        (change("optics", half_field_deg=0.15), r"half_field_deg = 0\.15 degrees make an image"),
+        (change("optics", efl_mm=0.05), r"efl_mm = 0\.05 make an image"),
+        (lambda t: t["vary"][0].update(low=9.0), r"vary\[0\]\.low must be <= high.* low = 9"),
+        (lambda t: t["vary"][0].update(surface=5), r"has 5 surfaces, 0\.\.4"),
+        (
+            lambda t: t["vary"].append(
+                {"kind": "curvature", "surface": 0, "low": 14.0, "high": 50.0}
+            ),
+            "cannot reach its rim.*1 / radius",
+        ),
+        (lambda t: t["vary"][0].update(colour=1), "known are configuration, high, kind, low"),
         (change("schedule", lens_rate="fast"), "must be a number"),
         (change("pixels", kernel_px=32), "odd"),
         (change("pixels", wavelengths_um=[0.5]), "three rows"),

@@ -49,6 +49,14 @@ def test_the_lens_is_held_at_first_and_frozen_at_last(recipe: DesignRecipe) -> N
     assert torch.equal(seen[3], seen[5])
 
 
+def test_without_a_network_the_lens_waits_for_none(recipe: DesignRecipe) -> None:
+    schedule = replace(recipe.schedule, hold_steps=2)
+    network = replace(recipe.network, name="", config={})
+    loop = make_loop(replace(recipe, schedule=schedule, network=network))
+    finish(loop, last_step=1)
+    assert bool(loop.parts.lens.moves.detach().any())
+
+
 def test_a_rate_of_zero_trains_the_network_alone(recipe: DesignRecipe) -> None:
     schedule = replace(recipe.schedule, lens_rate=0.0, hold_steps=0)
     loop = make_loop(replace(recipe, schedule=schedule))
@@ -136,6 +144,30 @@ def test_the_best_lens_is_kept_and_put_in_place(recipe: DesignRecipe) -> None:
     loop.take_best()
     assert loop.best_db == max([begin, *found])
     assert loop.judge().valid_db == loop.best_db
+
+
+def test_a_candidate_loses_to_none_that_was_measured_by_the_same_rule(
+    recipe: DesignRecipe,
+) -> None:
+    """The rule is PSNR less [limits]: a lens outside them may have more dB, and lose."""
+    schedule = replace(
+        recipe.schedule, lens_rate=0.3, hold_steps=2, steps=6, valid_steps=1, freeze_share=0.0
+    )
+    broken = replace(recipe, schedule=schedule, limits=replace(recipe.limits, min_bfl_mm=60.0))
+    loop = make_loop(broken)
+    first = loop.judge()
+    assert first.merit < first.valid_db
+    moments = [first, *loop.run(last_step=4)]
+    resumed = make_loop(broken)
+    resumed.load(loop.state())
+    moments += resumed.run()
+    merits = [moment.merit for moment in moments]
+    assert [moment.best_merit for moment in moments] == [
+        max(merits[: i + 1]) for i in range(len(merits))
+    ]
+    assert moments[-1].best_step == moments[merits.index(max(merits))].step
+    resumed.take_best()
+    assert resumed.judge().merit == max(merits)
 
 
 def test_with_weights_of_depths_the_least_loss_decides(table: dict[str, Any]) -> None:

@@ -71,6 +71,13 @@ def test_an_earlier_run_is_not_lost_by_mistake(recipe: DesignRecipe, tmp_path: P
         DesignRun(recipe, replace(options, resume=True))
 
 
+def test_a_start_without_light_is_refused_by_its_keys(recipe: DesignRecipe, tmp_path: Path) -> None:
+    pixels = replace(recipe.pixels, pitch_um=0.006)
+    with pytest.raises(ContractError, match=r"kernel_px\) of 0\.006 um \(pixels\.pitch_um\)"):
+        finish(replace(recipe, pixels=pixels), DesignOptions(out_dir=tmp_path))
+    assert not any(tmp_path.iterdir())
+
+
 def test_the_view_shows_fixed_patches(recipe: DesignRecipe, tmp_path: Path) -> None:
     view = finish(recipe, DesignOptions(out_dir=tmp_path), last_step=3).view()
     assert view.kernels.shape == (1, 3, 3, 33, 33)

@@ -170,10 +170,10 @@ def test_a_lens_that_is_to_stay_is_not_searched_for(
 @pytest.mark.parametrize(
     ("entry", "word"),
     [
-        ({"count": -1}, "counts >= 0"),
-        ({"spread": 1.5}, "counts >= 0"),
-        ({"dls_steps": -1}, "counts >= 0"),
-        ({"anywhere": 1.1}, "anywhere in 0..1"),
+        ({"count": -1}, "count must be >= 0; got -1"),
+        ({"spread": 1.5}, "spread must lie in 0..1; got 1.5"),
+        ({"dls_steps": -1}, "dls_steps must be >= 0; got -1"),
+        ({"anywhere": 1.1}, "anywhere must lie in 0..1"),
         ({"core_um": -1.0}, "core_um"),
         ({"merit": "area"}, "sum_abs"),
         ({"count": 8, "judged": 4}, "2 to 3 with a count of 8"),

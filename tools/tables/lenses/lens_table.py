@@ -27,8 +27,9 @@ from torch import Tensor, nn
 from camkit.errors import ContractError
 from camkit.models_def.design.assembly import field_azimuths, field_slopes, network_of, recorder_of
 from camkit.models_def.design.design_recipe import DesignRecipe, NetworkChoice, read_design
+from camkit.models_def.design.design_schedule import DesignSchedule
 from camkit.models_def.design.front import Front
-from camkit.models_def.design.loop import DesignLoop, DesignParts, DesignSchedule
+from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.loss import DesignLoss
 from camkit.models_def.optics.analysis.curves import axial_colour_mm
 from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens

@@ -375,7 +375,8 @@ def _text(report: dict[str, Any]) -> str:
         steps = [state[f"spot_rms_mm_{when}"] for when in ("before", "refocused", "after")]
         columns = [spots for spots in steps if spots is not None]
         fields = ", ".join(
-            " -> ".join(f"{1000 * mm:.1f}" for mm in row) for row in zip(*columns, strict=True)
+            f"{angle:.4g} degrees " + " -> ".join(f"{1000 * mm:.1f}" for mm in row)
+            for angle, *row in zip(state["field_angles_deg"], *columns, strict=True)
         )
         stages = "file -> refocused -> improved" if all(steps) else "file -> improved"
         efl = " -> ".join(dict.fromkeys(f"{state[f'efl_mm_{when}']:.4g}" for when in _WHEN))

@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from camkit.cli.design.design import is_picture_due
+from camkit.models_def.design.loop import DesignLoop
 
 RECIPE = """
 name = "tiny"
@@ -48,6 +49,35 @@ def test_a_design_leaves_lens_log_and_pictures_and_goes_on(camkit_command, tmp_p
     assert again.code == 2
     assert "--resume" in again.err
     assert camkit_command("lens", "convert", report["lens"], tmp_path / "tiny.zmx").code == 0
+
+
+def test_a_design_says_what_it_does(
+    camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recipe, out = tmp_path / "tiny.toml", tmp_path / "out"
+    text = RECIPE.replace("hold_steps = 0", "freeze_share = 1.0") + "[limits]\nmin_bfl_mm = 60.0\n"
+    recipe.write_text(text)
+    command = ("design", recipe, "--out-dir", out, "--steps", "4")
+    one_step = DesignLoop._one_step
+
+    def interrupted(loop: DesignLoop) -> float:
+        if loop.step == 3:
+            raise KeyboardInterrupt
+        return one_step(loop)
+
+    monkeypatch.setattr(DesignLoop, "_one_step", interrupted)
+    outcome = camkit_command(*command)
+    assert outcome.code == 130
+    lines = (
+        *("PSF by ", "times the Airy radius", "step 0: validation", "outside its [limits]"),
+        *("min_bfl_mm", "stays as it is in all 4 steps", "freeze_share (1)", "--resume"),
+    )
+    assert [line for line in lines if line not in outcome.err] == []
+    monkeypatch.undo()
+    outcome = camkit_command(*command, "--resume")
+    assert outcome.code == 0, outcome.err
+    assert "resumes at step 2 of 4" in outcome.err
+    assert "no lens was better than the one at the start" in outcome.out
 
 
 def test_resume_and_overwrite_exclude_each_other(camkit_command, tmp_path: Path) -> None:
