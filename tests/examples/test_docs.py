@@ -4,9 +4,7 @@ import json
 import re
 import shlex
 import subprocess
-import tomllib
 from collections.abc import Iterator, Sequence
-from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,16 +19,10 @@ from camkit.bundle.manifest import Manifest
 from camkit.cli.app import app
 from camkit.cli.exit_code import ExitCode
 from camkit.errors import CamkitError
-from camkit.models_def.design.design_recipe import TABLES, to_design
-from camkit.models_def.optics.configuration.configuration_table import ConfigurationTable
-from camkit.models_def.optics.search.improvement import RANGES
-from camkit.models_def.optics.search.variables import KINDS, PARAMETERS
 from camkit.runtime.machine import limits as machine_limits
 from camkit.runtime.machine.limits import Limit
 from camkit.runtime.output.sidecar import sidecar_path
 from tests.capture_factory import write_tiny_captures
-from tools.reference.__main__ import PAGES
-from tools.reference.recipe_page import EXAMPLE, attribute_texts
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -212,20 +204,6 @@ def test_results_are_data_and_pictures_of_no_great_size() -> None:
 
 def _reference(page: str) -> str:
     return (ROOT / "docs" / "reference" / f"{page}.md").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("page", PAGES)
-def test_generated_pages_are_what_the_code_says(page: str) -> None:
-    assert PAGES[page]() == _reference(page.removesuffix(".md")), "run `python -m tools.reference`"
-
-
-def test_the_page_of_recipes_explains_every_key_and_its_example_is_a_recipe() -> None:
-    for kind in (*TABLES.values(), ConfigurationTable):
-        texts = attribute_texts(kind)
-        assert list(texts) == [field.name for field in fields(kind)], kind
-        assert all(len(text.split()) > 1 and text.endswith(".") for text in texts.values()), kind
-    assert to_design(tomllib.loads(EXAMPLE)).prescription == "cooke-triplet"
-    assert {*RANGES} == {*KINDS} == {*PARAMETERS}
 
 
 def test_the_page_of_errors_names_every_exit_code_error_and_limit() -> None:

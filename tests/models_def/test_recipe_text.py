@@ -44,8 +44,8 @@ def test_what_a_key_is_comes_from_the_docstrings_of_a_class_and_its_bases() -> N
     notes = attribute_notes(BayerDataRecipe)
     assert notes["iso_max"] == "Highest ISO."
     # of a base, on two lines there
-    assert notes["picture_share"].startswith("Share of crops of pictures, the rest")
-    assert notes["picture_share"].endswith("every crop is procedural.")
+    assert notes["picture_share"].startswith("Share of crops from pictures, 0 to 1; the rest")
+    assert notes["picture_share"].endswith("without a folder of pictures, is procedural.")
 
 
 def test_what_is_no_table_is_refused() -> None:
