@@ -261,7 +261,7 @@ TABLES: Final[Mapping[str, type]] = {
     "camera": CameraChoice,
     "descent": Descent,
 }
-"""What the keys of each table of a recipe are read as; docs/reference/recipes.md lists them."""
+"""Classes that read the tables of a recipe; docs/reference/recipes.md lists their keys."""
 REPEATED: Final = frozenset({"vary", "phase"})
 """Tables that are written once for each number or phase."""
 REQUIRED: Final = ("name", "prescription", "vary", "optics", "pixels")

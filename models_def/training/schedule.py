@@ -1,10 +1,10 @@
-"""Options, learning rate, weight average and progress of a training run."""
+"""Options, result, learning rate, weight average and progress of a training run."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import torch
 from torch import Tensor
@@ -87,6 +87,42 @@ class TrainOptions:
             )
         if self.device != "cpu" and not torch.cuda.is_available():
             raise ContractError(f"device {self.device} is not there; use cpu")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainResult:
+    """The result of a run.
+
+    Attributes:
+        checkpoint: The last checkpoint.
+        log: The log.
+        steps: Steps done, earlier runs included.
+        elapsed_s: Wall time, earlier runs included.
+        cpu_s: CPU time, workers and earlier runs included.
+        baselines: What the network must beat: name -> validation dB.
+        valid_db: Of the weights that are exported.
+    """
+
+    checkpoint: Path
+    log: Path
+    steps: int
+    elapsed_s: float
+    cpu_s: float
+    baselines: Mapping[str, float]
+    valid_db: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the result as a flat mapping of plain values."""
+        flat = {f"{name}_db": db for name, db in self.baselines.items()}
+        return {
+            "checkpoint": str(self.checkpoint),
+            "log": str(self.log),
+            "steps": self.steps,
+            "elapsed_s": self.elapsed_s,
+            "cpu_s": self.cpu_s,
+            **flat,
+            "valid_db": self.valid_db,
+        }
 
 
 def progress_of(step: int, steps: int, by_time: float = 0.0) -> float:

@@ -4,8 +4,8 @@ pool of samples -> patches of a step -> network -> loss in the square-root domai
                                                         -> average of the weights -> validation
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -46,6 +46,7 @@ from camkit.models_def.training.refinement import Refinement
 from camkit.models_def.training.schedule import (
     NO_STEP,
     TrainOptions,
+    TrainResult,
     progress_of,
     short_time_text,
 )
@@ -56,42 +57,6 @@ __all__ = ["TrainOptions", "TrainResult", "checkpoint_path", "train"]
 
 LOG_STEPS: Final = 50
 Returned = TypeVar("Returned")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrainResult:
-    """The result of a run.
-
-    Attributes:
-        checkpoint: The last checkpoint.
-        log: The log.
-        steps: Steps done, earlier runs included.
-        elapsed_s: Wall time, earlier runs included.
-        cpu_s: CPU time, workers and earlier runs included.
-        baselines: What the network must beat: name -> validation dB.
-        valid_db: Of the weights that are exported.
-    """
-
-    checkpoint: Path
-    log: Path
-    steps: int
-    elapsed_s: float
-    cpu_s: float
-    baselines: Mapping[str, float]
-    valid_db: float
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the result as a flat mapping of plain values."""
-        flat = {f"{name}_db": db for name, db in self.baselines.items()}
-        return {
-            "checkpoint": str(self.checkpoint),
-            "log": str(self.log),
-            "steps": self.steps,
-            "elapsed_s": self.elapsed_s,
-            "cpu_s": self.cpu_s,
-            **flat,
-            "valid_db": self.valid_db,
-        }
 
 
 def train(

@@ -8,7 +8,6 @@ front.png       decibels gained against seconds: the front of methods
                 (`tools.methods`), else cameras of the measured bench
 """
 
-import argparse
 from pathlib import Path
 from typing import Final
 
@@ -17,6 +16,7 @@ import numpy as np
 
 from camkit.arrays import FloatArray
 from tools.methods.front_chart import RECORD, write_front_chart
+from tools.pictures.arguments import read_arguments
 from tools.pictures.captions import write_captioned, write_pixels
 from tools.pictures.views import VIEWS, View
 
@@ -28,15 +28,10 @@ NOTE: Final = "Simulated capture at 100 %. PSNR against the truth."
 
 def main() -> None:
     """Write the pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--out-dir", type=Path, default=Path("docs/images"))
-    parser.add_argument("cameras", nargs="*", default=list(VIEWS), metavar="CAMERA")
-    arguments = parser.parse_args()
-    out_dir: Path = arguments.out_dir
-    out_dir.mkdir(parents=True, exist_ok=True)
+    out_dir, cameras = read_arguments(__doc__.splitlines()[0], VIEWS, "CAMERA")
     total = 0
-    for number, name in enumerate(arguments.cameras):
-        print(f"{name} ({number + 1} of {len(arguments.cameras)}) ...", flush=True)
+    for number, name in enumerate(cameras):
+        print(f"{name} ({number + 1} of {len(cameras)}) ...", flush=True)
         view = VIEWS[name](name)
         for path in (_write_view(out_dir, name, view), _write_small(out_dir, name, view)):
             total += (size := path.stat().st_size)

@@ -8,7 +8,6 @@ moving-lamps.jpg    lamps that move: a bracket beside one exposure through a pla
 portable-chain.png  the graphs of `camkit portable`
 """
 
-import argparse
 import subprocess
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -40,6 +39,7 @@ from camkit.runtime.twin.simulate import SimulationOptions, photograph, write_ca
 from camkit.runtime.twin.truth import ideal_picture
 from camkit.scenes import named_scene
 from camkit.scenes.charts import LAMP_PITCH_PX, lamp_chart
+from tools.pictures.arguments import read_arguments
 from tools.pictures.captions import write_captioned
 from tools.pictures.crops import mosaic_sensor
 from tools.pictures.portable_chain import portable_chain
@@ -68,13 +68,8 @@ HEADING: Final = (
 
 def main() -> None:
     """Write the pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--out-dir", type=Path, default=Path("docs/images"))
-    parser.add_argument("pictures", nargs="*", default=list(PICTURES), metavar="PICTURE")
-    arguments = parser.parse_args()
-    out_dir: Path = arguments.out_dir
-    out_dir.mkdir(parents=True, exist_ok=True)
-    for name in arguments.pictures:
+    out_dir, pictures = read_arguments(__doc__.splitlines()[0], PICTURES, "PICTURE")
+    for name in pictures:
         path = out_dir / name
         with TemporaryDirectory() as folder:
             PICTURES[name](path, Path(folder))

@@ -47,7 +47,7 @@ DATA: Final = (
     ("tile_*", "warp*", "host joins tiles", "light", "(1, 3, h, w)"),
     ("warp*", 11.6, "host joins tiles", "picture", "(3, 512, 512)"),
 )
-"""What the host carries: from, to, what it does, name and shape."""
+"""Arrows of the host: from, to, what it does, name and shape of the data."""
 
 
 @chart

@@ -16,7 +16,7 @@ _AXES: Final = {
     **dict.fromkeys(("frames", "transient"), (3,)),
     "time_ps": (1,),
 }
-"""How many axes the arrays have that a page shows."""
+"""Numbers of axes that arrays may have to be shown, by name."""
 _COUNTS: Final = frozenset({"intensity", "frames", "transient"})
 
 

@@ -31,7 +31,7 @@ READ_AS: Final = (
     "Its codes are read by the colour space that the file states, else as sRGB; floats as linear "
     "light"
 )
-"""How a picture is read of which no sidecar says more."""
+"""Sentence on a picture of which no sidecar says more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

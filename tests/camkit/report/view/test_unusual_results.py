@@ -121,7 +121,7 @@ def _leaves(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]
 
 
 def test_an_edited_sidecar_is_read_or_refused_by_name(developed: Path, tmp_path: Path) -> None:
-    """Whatever value stands where another is expected, of every key that a page reads."""
+    """Put another value in every key that a page reads; none may end in a traceback."""
     record = json.loads(sidecar_path(developed).read_text())
     record["plan"] |= {
         "cells": {"side_px": 20, "rows": ["PFFF", "SWFF", "FFFF"]},
